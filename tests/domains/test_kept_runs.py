@@ -165,7 +165,7 @@ def test_the_world_of_a_store_that_was_deleted_makes_place_for_the_next(tmp_path
 
 
 def test_a_store_that_has_a_run_is_not_begun_anew(whole, planner):
-    with pytest.raises(InputError, match="has a run already; resume it by --resume"):
+    with pytest.raises(InputError, match="has a run already; the run has ended: take another file"):
         deploy(None, 3, 0.2, planner, store=whole[0])
 
 

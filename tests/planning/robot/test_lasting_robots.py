@@ -161,8 +161,8 @@ def test_texts_that_a_robot_prints_are_no_part_of_its_report(dsc):
 @pytest.mark.parametrize(
     ("target", "said"),
     [
-        ("unreadable.py", r"unreadable.py:2\)"),
-        ("unreadable:robot", r"unreadable.py:2\)"),
+        ("unreadable.py", "unreadable.py:2:11: "),
+        ("unreadable:robot", "unreadable.py:2:11: "),
         ("no_module:robot", "'no_module'"),
     ],
 )
