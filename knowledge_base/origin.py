@@ -60,33 +60,33 @@ def origin_of(text: str, source: str | None) -> Origin:
 
 
 class _Literal(NamedTuple):
-    """A text in a program, with its place and the lines of the program that contain it."""
+    """A text in a program: its line, its offset in this line in bytes, and the lines that contain it."""
 
     line: int
-    column: int
+    offset: int
     lines: Sequence[str]
 
     def origin(self, text: str, source: str) -> Origin:
         """Return the origin of the text, which has the same content as this literal."""
         written = [(number, one.strip(), one) for number, one in enumerate(text.split("\n")) if one.strip()]
-        first = written[0][0]
-        begins = next((number for number in range(len(self.lines)) if self._column_of(written[0][1], number) >= 0), 0)
-        columns = [self._column_of(content, begins + number - first) for number, content, _ in written]
+        first, start = written[0][0], len(self.lines[0].encode()[: self.offset].decode())
+
+        def column_of(content: str, number: int) -> int:
+            """Return the column, from 0, of a line of the text in a line of the program; -1 if it is missing."""
+            there = self.lines[number : number + 1]
+            return there[0].find(content, start if number == 0 else 0) if there else -1
+
+        begins = next((number for number in range(len(self.lines)) if column_of(written[0][1], number) >= 0), 0)
+        columns = [column_of(content, begins + number - first) for number, content, _ in written]
         if min(columns) < 0:  # e.g. a line break that is written as an escape
             return Origin(source, self.line, whole=True)
         shifts = [column - one.index(content) for column, (_, content, one) in zip(columns, written, strict=True)]
         own, later = (1, shifts[0]) if first else (shifts[0] + 1, next(iter(shifts[1:]), 0))
         return Origin(source, self.line + begins - first, own, later)
 
-    def _column_of(self, content: str, number: int) -> int:
-        """Return the column, from 0, of a line of the text in a line of the program; -1 if it is missing."""
-        if number >= len(self.lines):
-            return -1
-        return self.lines[number].find(content, self.column if number == 0 else 0)
-
 
 @lru_cache(maxsize=64)
-def _literals(file: str, changed: int, size: int) -> Mapping[str, tuple[_Literal, ...]]:  # noqa: ARG001  the file's state
+def _literals(file: str, changed: int, size: int) -> Mapping[str, Sequence[_Literal]]:  # noqa: ARG001  the file's state
     """Return the literals of a program by `_key`."""
     try:
         with tokenize.open(file) as stream:
@@ -94,13 +94,10 @@ def _literals(file: str, changed: int, size: int) -> Mapping[str, tuple[_Literal
         tree = parse_program(text)
     except (OSError, SyntaxError, ValueError, RecursionError, MemoryError):
         return {}
-    lines, found = text.splitlines(), dict[str, tuple[_Literal, ...]]()
+    lines, found = text.split("\n"), dict[str, list[_Literal]]()
     for node in _constants(tree):
-        key = _key(str(node.value))
-        last = node.end_lineno or node.lineno
-        column = len(lines[node.lineno - 1].encode()[: node.col_offset].decode())
-        literal = _Literal(node.lineno, column, lines[node.lineno - 1 : last])
-        found[key] = (*found.get(key, ()), literal)
+        literal = _Literal(node.lineno, node.col_offset, lines[node.lineno - 1 : node.end_lineno])
+        found.setdefault(_key(str(node.value)), []).append(literal)
     return found
 
 

@@ -20,6 +20,8 @@ from pathlib import Path
 
 from prose import WORDS
 
+from knowledge_base.origin import parse_program
+
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = ("knowledge_base", "dsc", "planning", "domains")
 LIMITS = Path(__file__).with_name("house.toml")
@@ -43,7 +45,7 @@ def code_lines(source: str) -> set[int]:
     """Return the numbers of the lines that have code: no comments, docstrings and blank lines."""
     strings = {
         line
-        for node in ast.walk(parse_source(source))
+        for node in ast.walk(parse_program(source))
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
         for line in range(node.lineno, (node.end_lineno or node.lineno) + 1)
     }
@@ -57,18 +59,10 @@ def imports(tree: ast.AST) -> list[ast.Import | ast.ImportFrom]:
     return [node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
 
 
-def parse_source(source: str) -> ast.Module:
-    """Return the syntax tree of a module."""
-    try:
-        return ast.parse(source)
-    except SystemError:  # finalizers that run during it confuse its counter (CPython issue 106905)
-        return ast.parse(source)
-
-
 def imported(file: Path, known: set[str]) -> set[str]:
     """Return the modules among `known` that a file imports, relative imports included."""
     found: set[str] = set()
-    for node in imports(parse_source(file.read_text("utf-8"))):
+    for node in imports(parse_program(file.read_text("utf-8"))):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names} & known
             continue
@@ -146,7 +140,7 @@ def banned_names(files: Iterable[Path]) -> dict[str, str]:
 
 def participles(files: Iterable[Path]) -> list[str]:
     """Return the functions whose whole name is a participle, instead of a verb with an object."""
-    trees = (parse_source(file.read_text("utf-8")) for file in files)
+    trees = (parse_program(file.read_text("utf-8")) for file in files)
     functions = (
         node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
     )
@@ -155,14 +149,14 @@ def participles(files: Iterable[Path]) -> list[str]:
 
 def clause_names() -> list[str]:
     """Return the tests whose name begins with a clause instead of a subject."""
-    trees = (parse_source(file.read_text("utf-8")) for file in modules("tests"))
+    trees = (parse_program(file.read_text("utf-8")) for file in modules("tests"))
     return [name for tree in trees for _, name in defined_names(tree) if _CLAUSE.match(name)]
 
 
 def _named(files: Iterable[Path]) -> Iterator[tuple[str, str]]:
     seen: set[str] = set()
     for file in files:
-        for line, name in defined_names(parse_source(file.read_text("utf-8"))):
+        for line, name in defined_names(parse_program(file.read_text("utf-8"))):
             if name not in seen:
                 seen.add(name)
                 yield name, f"{file.relative_to(ROOT)}:{line}"
@@ -173,9 +167,11 @@ def measures() -> dict[str, float]:
     product = modules(*SOURCES)
     sources = [file.read_text("utf-8") for file in product]
     code = [code_lines(source) for source in sources]
-    per_file = [sorted(set(_modules_of(parse_source(source)))) for source in sources]
+    per_file = [sorted(set(_modules_of(parse_program(source)))) for source in sources]
     import_lines = sum(
-        len({line for node in imports(parse_source(source)) for line in range(node.lineno, (node.end_lineno or 0) + 1)})
+        len(
+            {line for node in imports(parse_program(source)) for line in range(node.lineno, (node.end_lineno or 0) + 1)}
+        )
         for source in sources
     )
     lines = sum(map(len, code))

@@ -22,6 +22,7 @@ from dsc.deployment.model import parse_deployment
 from dsc.drawing import draw
 from dsc.monitoring.profile import parse_monitoring
 from dsc.text.profiles import parse_profile
+from knowledge_base.origin import parse_program
 from planning.engines.registry import engine
 
 ROOT = Path(__file__).parent.parent
@@ -151,7 +152,7 @@ def classes():
     found: dict[str, set[str]] = {}
     for package in PACKAGES:
         for path in (ROOT / package).rglob("*.py"):
-            for node in ast.walk(house.parse_source(path.read_text())):
+            for node in ast.walk(parse_program(path.read_text())):
                 if isinstance(node, ast.ClassDef):
                     body = {one.name for one in node.body if isinstance(one, ast.FunctionDef | ast.AsyncFunctionDef)}
                     found.setdefault(node.name, set()).update(body)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from inspect import getattr_static, iscoroutinefunction, isfunction, signature, unwrap
+from itertools import takewhile
 
 from dsc.components.component import Component
 from dsc.components.life_cycle import NEUTRAL, LifeCycle
@@ -51,7 +52,9 @@ def _hidden_names(component: Component) -> Iterator[str]:
             yield name
     if not hasattr(getattr_static(type(component), "mode", None), "__get__"):
         yield "mode"
-    for name in _METHODS:
+    own_kinds = takewhile(lambda kind: kind is not Component, type(component).__mro__)
+    own_names = set(vars(component)).union(*map(vars, own_kinds))
+    for name in filter(own_names.__contains__, _METHODS):  # a run checks its components, and the look-up is slow
         own = getattr_static(component, name, None)
         found = own if isinstance(own, property) else getattr(component, name, None)  # a property calls users' code
         if not callable(found) and not (name == "step" and component.period is None):
